@@ -44,10 +44,20 @@ Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
     return instance;
 }
 
+// How many geometries a bottom-level structure has that is queried itself. Where lanes are loaded for, it is the one that turns were told of
+// (trace/query_turns.glsl): what is the same for all lanes is not kept for each through all rounds.
+uint hedgerow_geometries_of_top(HedgerowRayQuery query) {
+    uint count = query.top_geometries;
+#ifdef HEDGEROW_LANES
+    if (HEDGEROW_ONE_LEVEL && HEDGEROW_ALL_BUILT) count = Structure(query.top).header.geometry_count;
+#endif
+    return count;
+}
+
 // The index of a meeting's geometry, and its first primitive. Where a bottom-level structure of one geometry is queried itself, nothing is loaded.
 uvec2 hedgerow_geometry_met(HedgerowRayQuery query, HedgerowMeeting met) {
     uvec2 index_and_first = uvec2(0u);
-    if (hedgerow_has_top(query) || query.top_geometries > 1u) {
+    if (hedgerow_has_top(query) || hedgerow_geometries_of_top(query) > 1u) {
         Instance instance = hedgerow_instance_of(query, met);
         HedgerowGeometry geometry = hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, met.primitive);
         index_and_first = uvec2(geometry.index, geometry.first);

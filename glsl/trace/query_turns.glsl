@@ -106,7 +106,11 @@ bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowT
     bool is_told = HEDGEROW_ALL_BUILT || any(notEqual(turns.told, uvec2(0u)));
     // Of one level the nodes and records of that structure are loaded by their indices.
     bool goes = turns.goes != 0u && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
-    if (is_told) waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);
+    if (is_told) {
+        waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);
+        // Rays into another one have ended. What a hit's geometry is asked of is loaded once for all lanes so.
+        if (HEDGEROW_ONE_LEVEL) query.top = turns.told;
+    }
     turns.ends |= goes && is_told ? 0u : turns.goes;
     turns.spent += turns.goes;
 #else

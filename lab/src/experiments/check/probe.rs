@@ -105,6 +105,16 @@ impl ProbeReport {
     }
 }
 
+/// What a probe is told of the structures that it queries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told {
+    Nothing,
+    /// `HEDGEROW_ONE_LEVEL`: they are bottom levels.
+    OneLevel,
+    /// `HEDGEROW_ALL_BUILT` as well: none is null or empty.
+    OneLevelBuilt,
+}
+
 /// A pipeline of its own, and its layout: neither of them ours.
 pub struct Probe {
     device: &'static Device,
@@ -125,9 +135,9 @@ impl Probe {
         Probe::of(device, &shaders::MEASURE_PROBE)
     }
 
-    /// The same for bottom levels alone (`HEDGEROW_ONE_LEVEL`).
+    /// The same for bottom levels alone.
     pub fn of_one_level(device: &'static Device) -> Probe {
-        Probe::with(device, &shaders::MEASURE_PROBE, Probe::GROUP, true)
+        Probe::with(device, &shaders::MEASURE_PROBE, Probe::GROUP, Told::OneLevel)
     }
 
     /// The same while another query of each ray goes on, into what turns would be told of. Each time the kind of what that has
@@ -142,13 +152,13 @@ impl Probe {
     }
 
     /// The same with loads lane by lane, where a subgroup is one that can, and the driver takes out what the pipeline's constants leave out:
-    /// SwiftShader does not, and follows the paths of sixteen lanes one by one (no end after 230 s). For bottom levels alone, or for both.
-    pub fn in_lanes(device: &'static Device, one_level: bool) -> Option<Probe> {
+    /// SwiftShader does not, and follows the paths of sixteen lanes one by one (no end after 230 s).
+    pub fn in_lanes(device: &'static Device, told: Told) -> Option<Probe> {
         let limits = &device.limits;
         let can = limits.subgroup_is_exact
             && limits.subgroup_size <= Loads::MAX_LANES
             && limits.driver != vk::DriverId::GOOGLE_SWIFTSHADER;
-        can.then(|| Probe::with(device, &shaders::MEASURE_PROBE_TURNS_LANES, limits.subgroup_size, one_level))
+        can.then(|| Probe::with(device, &shaders::MEASURE_PROBE_TURNS_LANES, limits.subgroup_size, told))
     }
 
     /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
@@ -156,11 +166,11 @@ impl Probe {
     /// # Panics
     /// The device does not take it.
     pub fn of(device: &'static Device, shader: &'static Shader) -> Probe {
-        Probe::with(device, shader, Probe::GROUP, false)
+        Probe::with(device, shader, Probe::GROUP, Told::Nothing)
     }
 
-    /// Of workgroups of `group`, which the shader may take as constants 0 and 4; and whether of one level, as constant 5.
-    fn with(device: &'static Device, shader: &'static Shader, group: u32, one_level: bool) -> Probe {
+    /// Of workgroups of `group`, which the shader may take as constants 0 and 4; what it is told are constants 5 and 6.
+    fn with(device: &'static Device, shader: &'static Shader, group: u32, told: Told) -> Probe {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("SPIR-V");
         let raw = device.ash_device();
         let range =
@@ -172,9 +182,9 @@ impl Probe {
                 .expect("a layout");
             let module =
                 raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).expect("a module");
-            let data = [group, u32::from(one_level)];
+            let data = [group, u32::from(told != Told::Nothing), u32::from(told == Told::OneLevelBuilt)];
             let entry = |(id, offset)| vk::SpecializationMapEntry { constant_id: id, offset, size: size_of::<u32>() };
-            let entries = [(0, 0), (4, 0), (5, 4)].map(entry);
+            let entries = [(0, 0), (4, 0), (5, 4), (6, 8)].map(entry);
             let constants = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::bytes_of(&data));
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)

@@ -5,7 +5,9 @@ use crate::experiments::check::agree::assert_agrees;
 use crate::experiments::check::backend::{Backend, Ours};
 use crate::experiments::check::cases::{Cases, Found, same};
 use crate::experiments::check::matrices::{Matrix, moved, rotation, scaled};
-use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, Probe, ProbeRay, ProbeReport, TERMINATE, flags};
+use crate::experiments::check::probe::{
+    CONFIRM, CONFIRM_ODD, IGNORE, Probe, ProbeRay, ProbeReport, TERMINATE, Told, flags,
+};
 use crate::experiments::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::experiments::check::world::{Part, World, inverse, transformed};
 use crate::random::SplitMix64;
@@ -124,7 +126,7 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
 /// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended, nor on how it loads.
 fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
     reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays, false)?;
-    let Some(in_lanes) = Probe::in_lanes(device, false) else { return Ok(()) };
+    let Some(in_lanes) = Probe::in_lanes(device, Told::Nothing) else { return Ok(()) };
     [Wide::Never, Wide::ByFlags, Wide::Always].into_iter().try_for_each(|wide| {
         let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
         reports_the_same(&Ours::with_options(device, options), &in_lanes, world, rays, true)
@@ -151,7 +153,8 @@ fn reports_the_same(ours: &Ours, probe: &Probe, world: &World, rays: &[ProbeRay]
 /// A shader for bottom levels alone reports of each part what another one does, and nothing of a top level.
 fn one_level(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
     let probe = Probe::of_one_level(device);
-    let in_lanes = Probe::in_lanes(device, true);
+    let in_lanes: Vec<Probe> =
+        [Told::OneLevel, Told::OneLevelBuilt].into_iter().filter_map(|told| Probe::in_lanes(device, told)).collect();
     for wide in [Wide::Never, Wide::Always] {
         let ours = Ours::with_options(device, AccelOptions { wide, ..AccelOptions::DEFAULT });
         let built = world.build(&ours);
@@ -162,13 +165,16 @@ fn one_level(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found
             let expected = ours.probe(part.structure, rays);
             same_reports("of one level", &probe.ask(parts[i], rays), &expected, rays)?;
             hits += expected.iter().filter(|report| report.committed.kind != 0).count();
-            let Some(in_lanes) = &in_lanes else { continue };
-            same_reports("of one level, lane by lane", &in_lanes.ask(parts[i], rays), &expected, rays)?;
-            for told in [parts[(i + 1) % parts.len()], top, 0] {
-                meets_nothing(
-                    &in_lanes.ask_told(parts[i], told, rays),
-                    "a part, lanes told of another structure or none,",
-                )?;
+            let others = [parts[(i + 1) % parts.len()], top, 0];
+            // None is no structure that is built.
+            for (in_lanes, others) in in_lanes.iter().zip([&others[..], &others[..2]]) {
+                same_reports("of one level, lane by lane", &in_lanes.ask(parts[i], rays), &expected, rays)?;
+                for &told in others {
+                    meets_nothing(
+                        &in_lanes.ask_told(parts[i], told, rays),
+                        "a part, lanes told of another structure or none,",
+                    )?;
+                }
             }
         }
         ensure!(hits > 20, "{hits} rays hit a part");
