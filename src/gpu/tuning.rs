@@ -216,7 +216,7 @@ impl Tuning {
                 workers: limits.workgroup_count.min(64),
                 small: 2048,
                 // Fast traces of 300 to 2,000 triangles take 0.25 to 0.7 of the time so, of 2,500 to 8,000 0.5 to 0.75 on two cores; top levels of
-                // 50 to 400 instances 0.25 to 0.85, of 2,400 to 8,000 entries 0.4 to 0.65, of 16,000 still 0.75, where more cores may do without.
+                // 50 to 400 instances 0.25 to 0.85, of 2,400 to 8,000 entries 0.4 to 0.7, of 16,000 still 0.8, where more cores may do without.
                 small_optimised: 8192,
                 // Of 600 to 1,000 triangles a fast trace takes 0.77 to 1.06 of the time so, of 1,500 and 2,000 on two cores 1.24.
                 small_hploc: 1024,
