@@ -10,8 +10,8 @@
 //   open    reads that list, histogram[round], near, the        writes entries, their gains and cuts, histogram[round + 1]
 //           structures below
 //
-// Weighing and opening are long: from the list, no invocation waits for another that opens one. How an entry is cut, and how its two parts
-// are, is found when it is weighed, and kept.
+// Weighing and opening take long. So what is opened is listed first: every invocation then has an entry to open, and none waits for another.
+// How an entry is cut, and how its two parts are, is found when it is weighed, and kept.
 //
 // What a round may spend is its share of what is left, so that the loosest entries are opened deeper than others are at all.
 // What lies beyond the fences of most entries (bvh/codes/quartiles.glsl) is opened last, as few rays come there, however large it is.
@@ -139,10 +139,10 @@ void rebraid_fences() {
     if (gl_LocalInvocationIndex == 0) state.near = near;
 }
 
-// What an entry begins at, as a part without a box of its own.
+// What an entry begins at, as a part without a box.
 Child part_of_entry(Entry entry) {
     uvec2 begin = begin_at(entry.start, entry.slots, entry.records);
-    return Child(entry.lo, begin.x, entry.hi, begin.y);
+    return Child(vec3(0), begin.x, vec3(0), begin.y);
 }
 
 // `Entry::cuts`: how it is cut, and how its two parts are, a byte each (cut_of()).
@@ -220,6 +220,7 @@ void open(uint i, uint behind, uint round) {
 }
 
 void rebraid_weigh(uint chunk) {
+    if (is_over(0u)) return;
     uvec2 range = range_of_chunk(0u, chunk);
     for (uint i = range.x + gl_LocalInvocationIndex; i < range.y; i += gl_WorkGroupSize.x) {
         Entry entry = entries.entry[i];

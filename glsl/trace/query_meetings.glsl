@@ -44,8 +44,8 @@ Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
     return instance;
 }
 
-// How many geometries a bottom-level structure has that is queried itself. Where lanes are loaded for, it is the one that turns were told of
-// (trace/query_turns.glsl): what is the same for all lanes is not kept for each through all rounds.
+// How many geometries a bottom-level structure has that is queried itself. With HEDGEROW_LANES it is the one that turns were told of
+// (trace/query_turns.glsl), the same for all lanes: loaded again, it is no number that each lane keeps through all rounds.
 uint hedgerow_geometries_of_top(HedgerowRayQuery query) {
     uint count = query.top_geometries;
 #ifdef HEDGEROW_LANES

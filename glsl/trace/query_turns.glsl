@@ -108,7 +108,7 @@ bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowT
     bool goes = turns.goes != 0u && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
     if (is_told) {
         waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);
-        // Rays into another one have ended. What a hit's geometry is asked of is loaded once for all lanes so.
+        // Rays into another structure have ended. So all lanes ask the same one for the geometry of a hit, and it is loaded once.
         if (HEDGEROW_ONE_LEVEL) query.top = turns.told;
     }
     turns.ends |= goes && is_told ? 0u : turns.goes;
