@@ -39,6 +39,10 @@ const LARGE: u32 = 4096;
 /// Entries of a top level that one node of eight holds: nothing comes of moving subtrees.
 const ONE_NODE: u32 = 8;
 
+/// Entries of a top level in nodes of eight up to which a quarter of a pass moves subtrees. Of more it takes longer than a driver's build, and rays
+/// meet 0.98 to 1.00 of what they do without (docs/notes/rays.md, "Many entries").
+const MANY_ENTRIES: u32 = 1 << 14;
+
 /// Records of wide structures, at most: what tracers can name of triangles, and fewer than the bits of an instance's record, above which
 /// slots of a node lie.
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
@@ -90,7 +94,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
     let unpaired = BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
         // Of two leaves there is nothing to move, and of those that are in one node of eight nothing comes of it.
-        optimise: if is_top { top_optimise(flags, is_wide) } else { bottom_optimise(flags, count) }
+        optimise: if is_top { top_optimise(flags, is_wide, count) } else { bottom_optimise(flags, count) }
             .filter(|_| count > if is_top && is_wide { ONE_NODE } else { 2 }),
         codes: Some(codes(flags, options, (is_top, is_wide), count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
@@ -129,17 +133,27 @@ pub(super) fn fewer_of_another_form(
     count: u32,
 ) -> impl Iterator<Item = u32> {
     let options = *options;
+    let entries_of = move |count| opened_to(flags, &options, count).unwrap_or(count);
     let made = move |count| match primitives {
         Primitives::Instances => {
-            let entries = opened_to(flags, &options, count).unwrap_or(count);
-            (entries <= ONE_NODE, is_wide(flags, &options, primitives, entries))
+            let entries = entries_of(count);
+            let is_wide = is_wide(flags, &options, primitives, entries);
+            (top_optimise(flags, is_wide, entries).filter(|_| entries > ONE_NODE).is_some(), is_wide)
         }
         _ => (is_quick(flags, count), is_wide(flags, &options, primitives, count)),
     };
+    // The most instances that have at most so many entries: one has one, and more have more.
+    let instances_of = |entries| {
+        let (mut least, mut most) = (1, entries);
+        while least < most {
+            let middle = u32::midpoint(least, most + 1);
+            if entries_of(middle) <= entries { least = middle } else { most = middle - 1 }
+        }
+        least
+    };
     let fewer = match primitives {
-        // The most instances whose entries are in one node.
-        Primitives::Instances => (1..ONE_NODE + 1).rev().find(|&fewer| made(fewer).0).into_iter().collect(),
-        _ => vec![FEW, LARGE - 1],
+        Primitives::Instances => [ONE_NODE, MANY_ENTRIES].map(instances_of),
+        _ => [FEW, LARGE - 1],
     };
     fewer.into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
 }
@@ -161,9 +175,10 @@ fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
 /// A top level has few entries and all rays go through it: most of a pass of reinsertion brings back more than it takes; with a whole one
 /// some take longer than a driver's. Of what becomes nodes of eight a quarter brings back as much. H-PLOC before that would not gain more,
 /// and a tree of opened instances less.
-fn top_optimise(flags: Flags, is_wide: bool) -> Option<ReinsertionOptions> {
+fn top_optimise(flags: Flags, is_wide: bool, entries: u32) -> Option<ReinsertionOptions> {
     let rounds = if is_wide { QUARTER_OF_A_PASS } else { MOST_OF_A_PASS };
-    (!flags.contains(Flags::PREFER_FAST_BUILD)).then_some(rounds)
+    let is_moved = !(is_wide && entries > MANY_ENTRIES);
+    (is_moved && !flags.contains(Flags::PREFER_FAST_BUILD)).then_some(rounds)
 }
 
 /// A fast build sorts by 8 bits less; low memory keeps codes in one word, which saves 8 bytes of scratch a primitive. What lies far from

@@ -105,8 +105,7 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
 
 #[test]
 fn what_the_flags_ask_for_is_what_the_host_builds() {
-    // Of the second as many that a fast trace is built by a chain of dispatches.
-    let [world, large] = [mixture(400, 3), mixture(2200, 5)];
+    let world = mixture(400, 3);
     let all = [
         Flags::empty(),
         REBRAID | Flags::PREFER_FAST_BUILD,
@@ -134,11 +133,25 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         assert_eq!(read.top.header().primitive_count > 400, opens, "{flags:?}");
         assert_eq!(entries_of(&read).values().any(|starts| starts.len() > 1), opens, "{flags:?}");
     }
+}
+
+/// More than one workgroup finishes, and so many that no subtrees are moved.
+#[test]
+fn fast_traces_of_many_entries_are_what_the_host_builds() {
     let (flags, options) = (Flags::PREFER_FAST_TRACE, AccelOptions::DEFAULT);
-    let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..large });
-    let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
-    assert!(read.top.header().primitive_count > 8192, "{} entries", read.top.header().primitive_count);
-    assert!(read.top.to_bytes() == expected.to_bytes(), "of many");
+    for (instances, at_least) in [(2200, 8193), (4400, 16_385)] {
+        let mut world = mixture(instances, 5);
+        // Two of them stand apart from all others, which have a node of their own.
+        for (i, x) in [(7, 9.0e4), (instances - 9, -8.0e4)] {
+            world.instances[i] = Instance::new(3, scaled(1.0, [x, 0.0, 0.0]));
+        }
+        let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..world });
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
+        let header = read.top.header();
+        assert!(header.primitive_count >= at_least, "{} entries", header.primitive_count);
+        assert_ne!(header.near_node, 0, "{instances} instances");
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{instances} instances");
+    }
 }
 
 #[test]
