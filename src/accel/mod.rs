@@ -26,7 +26,7 @@
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
 //! | none | H-PLOC, of over 2,048 primitives: of those measured the least time for a build and ten rays a triangle, 0.62 of an LBVH's (0.68 and 0.71 with three quarters of a pass of reinsertion and a whole one, 0.87 in nodes of two) | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 3.8 (2.2 in nodes of two) | 1.81 (1.19) |
-//! | `PREFER_FAST_TRACE` | H-PLOC and a pass of reinsertion, three quarters of one from 262,145 primitives on, one and a half up to 32,768, two up to 2,048 | the same as without, but for a quarter of a pass in nodes of eight, and opens instances ([`REBRAID`]) | 10.3 | 2.01 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and a pass of reinsertion, three quarters of one from 262,145 primitives on, one and a half up to 32,768, two up to 2,048 | the same as without, but for a quarter of a pass in nodes of eight, none over more than 16,384 entries, and opens instances ([`REBRAID`]) | 10.3 | 2.01 |
 //!
 //! H-PLOC begins with pairs of triangles that share an edge, in structures of over 2,048.
 //!
