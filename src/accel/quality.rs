@@ -39,8 +39,8 @@ const LARGE: u32 = 4096;
 /// Entries of a top level that one node of eight holds: nothing comes of moving subtrees.
 const ONE_NODE: u32 = 8;
 
-/// Entries of a top level in nodes of eight up to which a quarter of a pass moves subtrees. Of more it takes longer than a driver's build, and rays
-/// meet 0.985 to 1.00 of what they do without (docs/notes/rays.md, "Many entries").
+/// Entries of a top level in nodes of eight up to which a quarter of a pass moves subtrees. Over more, builds with it took up to twice as
+/// long as a driver's, and rays met 0.985 to 1.00 of what they meet without it (docs/notes/rays.md, "Many entries").
 const MANY_ENTRIES: u32 = 1 << 14;
 
 /// Records of wide structures, at most: what tracers can name of triangles, and fewer than the bits of an instance's record, above which
