@@ -18,7 +18,9 @@ const WITHOUT_TWIN: [(&str, &str); 8] = [
 ];
 
 /// What twins share, or a part of one, and is the plain form of no pass of its own.
-const SHARED_BY_TWINS: [&str; 12] = [
+const SHARED_BY_TWINS: [&str; 14] = [
+    "accel/parts",
+    "accel/world_box",
     "bvh/build",
     "bvh/clusters",
     "bvh/costs",

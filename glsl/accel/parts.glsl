@@ -2,7 +2,7 @@
 // is `Below` in src/accel/twin/mod.rs.
 //
 // A part is a Child. Of quantised nodes it is some of a node's slots, and `count` says which, a bit each. A part of one slot that holds a node
-// is that node, whole. Parts of a node do without a box of their own, which few need (box_around()).
+// is that node, whole. Only whole nodes have a box of their own: others have those in their slots.
 #ifndef HEDGEROW_ACCEL_PARTS
 #define HEDGEROW_ACCEL_PARTS
 #include "bvh/instances.glsl"
@@ -31,14 +31,22 @@ Child whole_part(Header header) {
     return root;
 }
 
+// How long the edges of a quantised node's cells are.
+vec3 cell_of(QuantisedNode node) {
+    uint e = node.exponents_and_nodes;
+    return uintBitsToFloat((uvec3(e, e >> 8, e >> 16) & 0xFFu) << 23);
+}
+
+// Of each axis the byte of a slot.
+vec3 bytes_of_slot(uvec2 bytes[3], uint slot) {
+    return vec3(byte_of_slot(bytes[0], slot), byte_of_slot(bytes[1], slot), byte_of_slot(bytes[2], slot));
+}
+
 // The box in a slot of a quantised node.
 Box box_in_slot(QuantisedNode node, uint slot) {
-    uint e = node.exponents_and_nodes;
-    vec3 cell = uintBitsToFloat((uvec3(e, e >> 8, e >> 16) & 0xFFu) << 23);
-    vec3 lo = vec3(byte_of_slot(node.lo[0], slot), byte_of_slot(node.lo[1], slot), byte_of_slot(node.lo[2], slot));
-    vec3 hi = vec3(byte_of_slot(node.hi[0], slot), byte_of_slot(node.hi[1], slot), byte_of_slot(node.hi[2], slot));
-    precise vec3 least = uintBitsToFloat(node.origin) + lo * cell;
-    precise vec3 greatest = uintBitsToFloat(node.origin) + hi * cell;
+    vec3 cell = cell_of(node);
+    precise vec3 least = uintBitsToFloat(node.origin) + bytes_of_slot(node.lo, slot) * cell;
+    precise vec3 greatest = uintBitsToFloat(node.origin) + bytes_of_slot(node.hi, slot) * cell;
     return Box(least, greatest);
 }
 
@@ -80,14 +88,6 @@ Child part_of_node(QuantisedNode node, uint index, uint slots) {
         part = Child(b.lo, node.first_child + rank_of_node(nodes, slot), b.hi, ALL_SLOTS);
     }
     return part;
-}
-
-// The box around a part of `node`.
-Box box_around(QuantisedNode node, Child part) {
-    if (part.count == ALL_SLOTS) return Box(part.lo, part.hi);
-    Box b = empty_box();
-    for (uint left = part.count; left != 0u; left &= left - 1u) b = united(b, box_in_slot(node, uint(findLSB(left))));
-    return b;
 }
 
 // How large a box is in the world, whichever way its instance turns it: about the square of the sum of its edges. By its own area two long
@@ -180,27 +180,33 @@ uint cut_of(QuantisedNode node, uint slots, Child part) {
     return others;
 }
 
-// The children of a node of two; of what cannot be opened twice itself, and false.
-bool open_node_of_two(Structure structure, uint slots, Child child, out Child children[2]) {
-    bool opens = child.count == 0u && child.index < (slots & INDEX_MASK);
+bool is_node_of_two(uint slots, Child child) {
+    return child.count == 0u && child.index < (slots & INDEX_MASK);
+}
+
+// The children of a node of two; of what is none twice itself.
+void open_node_of_two(Structure structure, uint slots, Child child, out Child children[2]) {
     children[0] = child;
     children[1] = child;
-    if (opens) {
+    if (is_node_of_two(slots, child)) {
         Node node = structure.nodes[child.index];
         children[0] = node.left;
         children[1] = node.right;
     }
-    return opens;
 }
 
-// The two parts of a part of either form, which cut_of() cuts by `cut`; of what cannot be opened twice itself, and false.
-bool open_part(Structure structure, QuantisedNode node, uint slots, Child part, uint cut, out Child parts[2]) {
-    if ((slots & FORM_QUANTISED) == 0u) return open_node_of_two(structure, slots, part, parts);
-    parts[0] = part;
-    parts[1] = part;
-    if (cut == 0u) return false;
-    parts[0] = part_of_node(node, part.index, part.count & slots_in_use(node) & ~cut);
-    parts[1] = part_of_node(node, part.index, cut);
-    return true;
+// Whether a part of either form can be opened, which cut_of() cuts by `cut`.
+bool opens(uint slots, Child part, uint cut) {
+    return (slots & FORM_QUANTISED) != 0u ? cut != 0u : is_node_of_two(slots, part);
+}
+
+// The two parts of one that can be opened.
+void open_part(Structure structure, QuantisedNode node, uint slots, Child part, uint cut, out Child parts[2]) {
+    if ((slots & FORM_QUANTISED) == 0u) {
+        open_node_of_two(structure, slots, part, parts);
+    } else {
+        parts[0] = part_of_node(node, part.index, part.count & slots_in_use(node) & ~cut);
+        parts[1] = part_of_node(node, part.index, cut);
+    }
 }
 #endif

@@ -3,15 +3,15 @@
 // src/accel/twin/mod.rs is the twin.
 //
 //   fences  reads entries; one workgroup                        writes the sample, near
-//   weigh   reads entries, near, the structures below           writes gains and cuts of all entries, histogram[0]
+//   weigh   reads entries, near, the structures below           writes gains of all entries, how they are cut, histogram[0]
 //   select  reads gains, histogram[round]                       writes sums[chunk]: entries that the round opens
 //   list    reads gains, histogram[round], sums                 writes count[round + 1]; in place of the gains of the entries
 //                                                               that come to be, the numbers of those that are opened
-//   open    reads that list, histogram[round], near, the        writes entries, their gains and cuts, histogram[round + 1]
+//   open    reads that list, histogram[round], near, the        writes entries, their gains, how they are cut, histogram[round + 1]
 //           structures below
 //
-// Weighing and opening take long. So what is opened is listed first: every invocation then has an entry to open, and none waits for another.
-// How an entry is cut, and how its two parts are, is found when it is weighed, and kept.
+// Opening takes long. So what is opened is listed first: every invocation then has an entry to open, and none waits for another. The boxes
+// that an entry's own is made of also say what opening it saves; how it is cut is found for that, and kept.
 //
 // What a round may spend is its share of what is left, so that the loosest entries are opened deeper than others are at all.
 // What lies beyond the fences of most entries (bvh/codes/quartiles.glsl) is opened last, as few rays come there, however large it is.
@@ -145,49 +145,10 @@ Child part_of_entry(Entry entry) {
     return Child(vec3(0), begin.x, vec3(0), begin.y);
 }
 
-// `Entry::cuts`: how it is cut, and how its two parts are, a byte each (cut_of()).
-uint cut_in(uint cuts, uint at) {
-    return cuts >> 8u * at & 0xFFu;
-}
-
-// The area that rays need not enter any more for each entry more, if the entry over a part of `node` is opened once, or its children too:
-// from the eight boxes below it, transformed. Completes `entry.cuts`.
-uint gain_of(inout Entry entry, vec4 m[3], Structure structure, QuantisedNode node) {
-    uint slots = entry.slots;
-    Child opened = part_of_entry(entry);
-    if (entry.cuts == 0u) entry.cuts = cut_of(node, slots, opened);
-    Child children[2];
-    if (!open_part(structure, node, slots, opened, cut_in(entry.cuts, 0), children)) return NO_GAIN;
-    Box whole = empty_box();
-    precise float halves = 0.0, quarters = 0.0;
-    float added = 1.0;
-    for (uint side = 0; side < 2; ++side) {
-        QuantisedNode of_child = node_of(structure, slots, children[side], opened.index, node);
-        uint cut = cut_of(of_child, slots, children[side]);
-        entry.cuts |= cut << 8u * (side + 1u);
-        Child grandchildren[2];
-        bool opens = open_part(structure, of_child, slots, children[side], cut, grandchildren);
-        Box part = empty_box();
-        precise float pieces = 0.0;
-        for (uint quarter = 0; quarter < 2; ++quarter) {
-            QuantisedNode below = node_of(structure, slots, grandchildren[quarter], children[side].index, of_child);
-            Box piece = box_of_children(m, structure, below, slots, grandchildren[quarter]);
-            pieces += half_area(piece);
-            part = united(part, piece);
-        }
-        float area = half_area(part);
-        halves += area;
-        quarters += opens ? pieces : area;
-        added += opens ? 1.0 : 0.0;
-        whole = united(whole, part);
-    }
-    float area = half_area(whole);
-    precise float once = area - halves;
-    // By a constant: division may be inexact.
-    precise float twice = (area - quarters) * (added == 3.0 ? 1.0 / 3.0 : added == 2.0 ? 0.5 : 1.0);
-    float gain = max(once, twice);
-    if (!(gain > 0.0) || !is_finite(vec3(area))) return NO_GAIN;
-    return floatBitsToUint(is_apart(Box(entry.lo, entry.hi), state.near) ? min(gain, FAR_GAIN) : gain);
+// What opening an entry to these halves saves.
+uint gain_of(Entry entry, Halves halves) {
+    if (!(halves.saved > 0.0) || !is_finite(vec3(halves.saved))) return NO_GAIN;
+    return floatBitsToUint(is_apart(Box(entry.lo, entry.hi), state.near) ? min(halves.saved, FAR_GAIN) : halves.saved);
 }
 
 void count_gain(uint gain, uint round) {
@@ -199,23 +160,27 @@ void open(uint i, uint behind, uint round) {
     Entry parent = entries.entry[i];
     GivenInstance given = instance_of(parent);
     Structure structure = Structure(given.structure);
+    uint slots = parent.slots;
     Child opened = part_of_entry(parent);
-    QuantisedNode node = node_of(structure, parent.slots, opened);
+    QuantisedNode node = node_of(structure, slots, opened);
+    bool is_last = round + 1u == ROUNDS;
     Child parts[2];
     // What has a gain can be opened.
-    open_part(structure, node, parent.slots, opened, cut_in(parent.cuts, 0), parts);
+    open_part(structure, node, slots, opened, parent.cut, parts);
     for (uint side = 0; side < 2; ++side) {
         uint to = side == 0u ? i : behind;
-        QuantisedNode of_part = node_of(structure, parent.slots, parts[side], opened.index, node);
-        Box b = world_box(given.to_world, structure, of_part, parent.slots, parts[side]);
-        Entry entry = entry_over(b, parent.instance, parts[side], parent.slots, parent.records, parent.given);
-        entry.cuts = cut_in(parent.cuts, side + 1u);
-        if (round + 1u < ROUNDS) {
-            uint gain = gain_of(entry, given.to_world, structure, of_part);
+        QuantisedNode of_part = node_of(structure, slots, parts[side], opened.index, node);
+        uint cut = is_last ? 0u : cut_of(of_part, slots, parts[side]);
+        Halves halves = halves_of(given.to_world, structure, of_part, slots, parts[side], cut);
+        Box b = united(halves.of[0], halves.of[1]);
+        Entry entry = entry_over(b, parent.instance, parts[side], slots, parent.records, parent.given);
+        entry.cut = cut;
+        entries.entry[to] = entry;
+        if (!is_last) {
+            uint gain = opens(slots, parts[side], cut) ? gain_of(entry, halves) : NO_GAIN;
             gains.word[to] = gain;
             count_gain(gain, round + 1u);
         }
-        entries.entry[to] = entry;
     }
 }
 
@@ -228,9 +193,13 @@ void rebraid_weigh(uint chunk) {
         if (entry.left_out == 0u) {
             GivenInstance given = instance_of(entry);
             Structure structure = Structure(given.structure);
-            QuantisedNode node = node_of(structure, entry.slots, part_of_entry(entry));
-            gain = gain_of(entry, given.to_world, structure, node);
-            entries.entry[i].cuts = entry.cuts;
+            Child part = part_of_entry(entry);
+            QuantisedNode node = node_of(structure, entry.slots, part);
+            uint cut = cut_of(node, entry.slots, part);
+            if (opens(entry.slots, part, cut)) {
+                gain = gain_of(entry, halves_of(given.to_world, structure, node, entry.slots, part, cut));
+                entries.entry[i].cut = cut;
+            }
         }
         gains.word[i] = gain;
         count_gain(gain, 0u);

@@ -23,7 +23,7 @@ struct Entry {
     uint records;
     uvec2 given;              // address of the GivenInstance
     uint left_out;            // 0, or why it is
-    uint cuts;                // how re-braiding cuts it (accel/parts.glsl), or 0: that is not known yet
+    uint cut;                 // what re-braiding cuts off of it, once it is weighed (accel/parts.glsl, cut_of())
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer GivenInstances { GivenInstance instance[]; };

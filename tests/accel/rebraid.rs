@@ -139,7 +139,7 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
 #[test]
 fn fast_traces_of_many_entries_are_what_the_host_builds() {
     let (flags, options) = (Flags::PREFER_FAST_TRACE, AccelOptions::DEFAULT);
-    for (instances, at_least) in [(2200, 8193), (4400, 16_385)] {
+    for (instances, at_least) in [(2400, 8193), (4800, 16_385)] {
         let mut world = mixture(instances, 5);
         // Two of them stand apart from all others, which have a node of their own.
         for (i, x) in [(7, 9.0e4), (instances - 9, -8.0e4)] {

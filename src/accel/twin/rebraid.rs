@@ -34,7 +34,10 @@ pub fn rebraid<'a>(
             let (entry, instance) = (entries[i], of(&entries[i]));
             let Some(below) = below(instance.structure) else { continue };
             let Some(children) = below.opened(&entry.start) else { continue };
-            let [left, right] = children.map(|c| below.entry_over(entry.instance, &instance.transform, c));
+            let [left, right] = children.map(|start| {
+                let halves = below.halves(&instance.transform, &start);
+                Entry { bounds: Ok(halves.union()), start, ..entry }
+            });
             entries[i] = left;
             entries.push(right);
         }
@@ -42,25 +45,10 @@ pub fn rebraid<'a>(
 }
 
 impl Below<'_> {
-    /// The area that is saved for each entry more, if the entry is opened once, or its children too.
+    /// What opening an entry saves.
     fn gain_of(&self, entry: &Entry, m: &[[f32; 4]; 3]) -> Option<f32> {
-        let children = self.opened(&entry.start)?;
-        let whole = self.fine_box(m, entry.start, 3).half_area();
-        let halves = children.map(|child| self.fine_box(m, child, 2).half_area());
-        let mut quarters = 0.0;
-        let mut added = 1;
-        for (child, half) in children.iter().zip(halves) {
-            quarters += match self.opened(child) {
-                Some([a, b]) => {
-                    added += 1;
-                    self.fine_box(m, a, 1).half_area() + self.fine_box(m, b, 1).half_area()
-                }
-                None => half,
-            };
-        }
-        let once = whole - (halves[0] + halves[1]);
-        let twice = (whole - quarters) * [1.0, 0.5, 1.0 / 3.0][added - 1];
-        let gain = once.max(twice);
-        (whole.is_finite() && gain > 0.0).then_some(gain)
+        self.opened(&entry.start)?;
+        let saved = self.halves(m, &entry.start).saved;
+        (saved.is_finite() && saved > 0.0).then_some(saved)
     }
 }
