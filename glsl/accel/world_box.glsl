@@ -45,8 +45,9 @@ struct WorldGrid {
 };
 
 WorldGrid grid_in_world(vec4 m[3], QuantisedNode node) {
-    // Above the nine roundings between here and box_in_grid(), each of them 2^-24 of all that is added.
-    const float SLACK = uintBitsToFloat((127u - 20u) << 23);
+    // Until box_in_grid() has added all, what begins at the origin is rounded six times and what is stepped four times, each time by 2^-24 of it
+    // at most, and a box reaches over at most 255 steps: 8 and 128 * 8 such parts hold that.
+    const float SLACK = uintBitsToFloat((127u - 21u) << 23);
     vec3 cell = cell_of(node);
     WorldGrid grid;
     for (uint row = 0; row < 3; ++row) {
@@ -54,7 +55,7 @@ WorldGrid grid_in_world(vec4 m[3], QuantisedNode node) {
         precise vec3 step = m[row].xyz * cell;
         vec3 size = abs(from), far = abs(step);
         precise float at = ((from.x + from.y) + from.z) + m[row].w;
-        precise float slack = SLACK * ((((size.x + size.y) + size.z) + abs(m[row].w)) + 256.0 * ((far.x + far.y) + far.z));
+        precise float slack = SLACK * ((((size.x + size.y) + size.z) + abs(m[row].w)) + 128.0 * ((far.x + far.y) + far.z));
         precise float below = at - slack;
         precise float above = at + slack;
         grid.below[row] = below;

@@ -107,7 +107,7 @@ struct WorldGrid {
 
 impl WorldGrid {
     fn new(m: &[[f32; 4]; 3], node: &QuantisedNode) -> WorldGrid {
-        let slack_of_size = 2f32.powi(-20);
+        let slack_of_size = 2f32.powi(-21);
         let (origin, cell) = node.grid();
         let sum = |[x, y, z]: [f32; 3]| (x + y) + z;
         let mut grid = WorldGrid { below: [0.0; 3], above: [0.0; 3], step: [[0.0; 3]; 3] };
@@ -117,7 +117,7 @@ impl WorldGrid {
             let step: [f32; 3] = std::array::from_fn(|k| axes[k] * cell[k]);
             let at = sum(from) + w;
             let size = sum(from.map(f32::abs)) + w.abs();
-            let slack = slack_of_size * (size + 256.0 * sum(step.map(f32::abs)));
+            let slack = slack_of_size * (size + 128.0 * sum(step.map(f32::abs)));
             grid.below[row] = at - slack;
             grid.above[row] = at + slack;
             grid.step[row] = step;
