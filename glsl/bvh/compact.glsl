@@ -5,7 +5,7 @@
 //   sizes    reads and writes places
 //   indices  reads and writes places, those of large subtrees
 //   nodes    reads the source and places        writes the target's header and nodes
-//   records  reads the source                   writes the target's records, over the places, and table of geometries
+//   records  reads the source                   writes the target's records, over the places, and what lies behind them
 //
 // A node's index in the target is the way to it from the root: a left child is one behind its parent, a right child one and
 // the left one's subtree. Climbing to the root from each node took most of the time, so it is done for the roots of large

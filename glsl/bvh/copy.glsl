@@ -67,12 +67,15 @@ Header compacted(Header header) {
         header.root = empty_root();
         header.active_count = 0;
         header.inner_nodes = 0;
+        header.near_node = 0;
+        header.far_sides = 0;
     }
     header.primitive_count = header.active_count;
     header.pairs = min(header.pairs, header.active_count);
     header.node_slots = max(header.inner_nodes, 1);
-    // A root that is a node is the first.
+    // A root that is a node is the first. What is near is its left child.
     if (header.root.count == 0) header.root.index = 0;
+    if (header.near_node != 0) header.near_node = 1;
     return header;
 }
 #endif

@@ -109,7 +109,7 @@ struct Header {
     uint split_from;
     uint child_order;         // 1: left children are those that rays look into first that end at any hit
     uint pairs;               // of quantised trees of triangles: records that hold two
-    uint near_node;           // of a quantised top level with something far: the node over what is not; otherwise 0
+    uint near_node;           // of a top level with something far: the node over what is not; otherwise 0
     uint far_sides;           // on which sides of that node something is: bits 2 * axis, and 1 more on the positive side
     uint reserved[4];
 };

@@ -6,7 +6,7 @@
 //   search   reads nodes, parents               writes moves, gains
 //   match    reads parents, moves, gains        writes firsts
 //   settle   reads parents, moves, firsts       writes moves: only those that are made are left
-//   move     reads moves                        writes nodes, parents; the header: children have no order any more
+//   move     reads moves                        writes nodes, parents; the header: children have no order any more, and nothing is told of what is far
 //
 //   alone    all of that in all rounds, by one workgroup, for a small tree
 //

@@ -364,11 +364,9 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.is_prepared = 1u;
     if (hedgerow_prepare_for(hedgerow_is_in_top(query), ray, query.prepared) && goes && !skips) {
         hedgerow_begin_at(query, root.x, root.y);
-        if (hedgerow_is_quantised(query)) {
-            hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
-            bool may_begin_near = hedgerow_is_in_top(query) && near != 0u;
-            if (may_begin_near && !hedgerow_meets_far(query, FarBoxes(far), far_sides)) query.index = near;
-        }
+        if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
+        bool may_begin_near = hedgerow_is_in_top(query) && near != 0u;
+        if (may_begin_near && !hedgerow_meets_far(query, FarBoxes(far), far_sides)) query.index = near;
 #ifdef HEDGEROW_LINK_COUNTS
         if (!hedgerow_is_in_top(query)) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif

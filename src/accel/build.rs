@@ -6,6 +6,7 @@ use super::rebraid::Rebraid;
 use super::{AccelOptions, quality};
 use crate::bvh::builder::{BuildJob, BuildOptions, Builder};
 use crate::bvh::codes::Codes;
+use crate::bvh::far;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::layout::NODES_OFFSET;
 use crate::bvh::refit::{self, Refit};
@@ -153,7 +154,10 @@ impl Build {
             Some(wide) => {
                 Sizes { structure: wide.structure, scratch: before + builder.scratch.max(wide.scratch), ..builder }
             }
-            None => Sizes { scratch: before + builder.scratch, ..builder },
+            None => {
+                let far = if self.is_top() { far::BYTES } else { 0 };
+                Sizes { structure: builder.structure + far, scratch: before + builder.scratch, ..builder }
+            }
         }
     }
 
@@ -213,7 +217,9 @@ impl Build {
 
     /// What must run behind the builder's part, with a barrier before.
     pub fn epilogue(&self, structure: Region, scratch: Region) -> Result<Vec<Step>> {
-        let Some(wide) = &self.wide else { return Ok(Vec::new()) };
+        let Some(wide) = &self.wide else {
+            return Ok(self.is_top().then(|| far::step(structure.address, false)).into_iter().collect());
+        };
         let parts = self.scratch(0);
         let source = scratch.behind(parts.binary).address;
         if !self.numbered {
@@ -241,6 +247,10 @@ impl Build {
             structure,
             scratch: scratch.behind(self.scratch(0).builder),
         }
+    }
+
+    fn is_top(&self) -> bool {
+        self.given.primitives() == Primitives::Instances
     }
 
     fn input(&self, scratch: u64) -> Input {

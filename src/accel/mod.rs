@@ -101,9 +101,8 @@ pub struct AccelOptions {
     pub rebraid_budget: f32,
     /// The codes that bottom levels are sorted by; `None` takes [`Codes::for_count`]. Flags do not change those that are given.
     pub bottom_codes: Option<Codes>,
-    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust),
-    /// in nodes of eight [`CodeBounds::Apart`](crate::bvh::codes::CodeBounds::Apart), as an instance far from the others would put them
-    /// all into one cell, and with as many bits as the device finds that the instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
+    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Apart`](crate::bvh::codes::CodeBounds::Apart),
+    /// as an instance far from the others would put them all into one cell, and with as many bits as the device finds that the instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
     pub top_codes: Option<Codes>,
     /// Which structures get nodes of eight children.
     pub wide: Wide,

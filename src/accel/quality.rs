@@ -96,7 +96,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         // Of two leaves there is nothing to move, and of those that are in one node of eight nothing comes of it.
         optimise: if is_top { top_optimise(flags, is_wide, count) } else { bottom_optimise(flags, count) }
             .filter(|_| count > if is_top && is_wide { ONE_NODE } else { 2 }),
-        codes: Some(codes(flags, options, (is_top, is_wide), count)),
+        codes: Some(codes(flags, options, is_top, count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
         collapse: if is_top { Collapse::OFF } else { collapse(flags, is_wide) },
@@ -182,18 +182,14 @@ fn top_optimise(flags: Flags, is_wide: bool, entries: u32) -> Option<Reinsertion
 }
 
 /// A fast build sorts by 8 bits less; low memory keeps codes in one word, which saves 8 bytes of scratch a primitive. What lies far from
-/// the others would put them all into one cell of a top level: its bounds are robust, and where it becomes nodes of eight, that is apart.
-fn codes(flags: Flags, options: &AccelOptions, (is_top, is_wide): (bool, bool), count: u32) -> Codes {
+/// the others would put them all into one cell of a top level: its bounds are robust, with what is far apart, so that rays begin at the rest.
+fn codes(flags: Flags, options: &AccelOptions, is_top: bool, count: u32) -> Codes {
     if let Some(codes) = if is_top { options.top_codes } else { options.bottom_codes } {
         return codes;
     }
     let codes = Codes::for_count(count);
     let bits = if flags.contains(Flags::PREFER_FAST_BUILD) { codes.bits.saturating_sub(8).max(8) } else { codes.bits };
-    let bounds = match (is_top, is_wide) {
-        (false, _) => CodeBounds::Full,
-        (true, false) => CodeBounds::Robust,
-        (true, true) => CodeBounds::Apart,
-    };
+    let bounds = if is_top { CodeBounds::Apart } else { CodeBounds::Full };
     Codes { bounds, ..codes }.with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
 }
 

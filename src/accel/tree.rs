@@ -15,9 +15,9 @@ pub enum Tree<R: Record> {
 }
 
 impl<R: Record> Tree<R> {
-    /// In the form that is asked for.
+    /// In the form that is asked for; of a top level with what is far told.
     pub(crate) fn of(tree: Bvh2<R>, is_wide: bool) -> Tree<R> {
-        if is_wide { Tree::OfEight(Wide8q::of(&tree)) } else { Tree::OfTwo(tree) }
+        if is_wide { Tree::OfEight(Wide8q::of(&tree)) } else { Tree::OfTwo(tree.with_far_told()) }
     }
 
     /// Takes a structure's bytes apart; what lies behind them is of no interest.

@@ -8,14 +8,15 @@
 //! | [`Node`] × `node_slots` | 64 each | [`NODES_OFFSET`] |
 //! | [`Record`] × `primitive_count` | 40, 28 or 128 each | behind the nodes: [`BvhOffsets::records_offset`] |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
+//! | [`Aabb`] × 6, of a top level that has something far ([`super::far`]) | 24 each | behind the records |
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` records from `index` on, in the *primitive order*,
 //! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`InstanceRecord`]s. A slot that no child
 //! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
 //! `active` − 1 on are unused.
 
+use super::far;
 use super::wide::Form;
-use super::wide::far;
 use super::wide::pairs::SAVED_BY_PAIR;
 use super::wide::quantised::QuantisedNode;
 use crate::geometry::Aabb;
@@ -373,7 +374,7 @@ pub struct Header {
     pub child_order: u32,
     /// Of a quantised tree of triangles: records that hold two ([`super::wide::pairs`]). Otherwise 0.
     pub pairs: u32,
-    /// Of a quantised top level that has something far ([`super::wide::far`]): the node over what is not, where rays begin that meet nothing
+    /// Of a top level that has something far ([`super::far`]): the node over what is not, where rays begin that meet nothing
     /// far. Otherwise 0.
     pub near_node: u32,
     /// On which sides of that node something is: a bit each.
@@ -493,6 +494,8 @@ pub struct Bvh2<R: Record = Triangle> {
     pub records: Vec<R>,
     /// The table of geometries; empty where there is one.
     pub geometries: Vec<GeometryEntry>,
+    /// The boxes of what is far, by sides; empty where nothing is.
+    pub far: Vec<Aabb>,
 }
 
 impl<R: Record> Bvh2<R> {
@@ -508,12 +511,14 @@ impl<R: Record> Bvh2<R> {
             let what = format!("{has} bytes, {} primitives need {needs}", header.primitive_count);
             return Err(Error::InvalidStructure(what));
         }
+        let far = offsets.bytes - far::bytes(&header);
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
         Ok(Bvh2 {
             header,
             nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, offsets.records_offset)),
             records: bytemuck::pod_collect_to_vec(part(offsets.records_offset, offsets.geometries_offset)),
-            geometries: bytemuck::pod_collect_to_vec(part(offsets.geometries_offset, offsets.bytes)),
+            geometries: bytemuck::pod_collect_to_vec(part(offsets.geometries_offset, far)),
+            far: bytemuck::pod_collect_to_vec(part(far, offsets.bytes)),
         })
     }
 
@@ -523,6 +528,7 @@ impl<R: Record> Bvh2<R> {
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.records));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.far));
         bytes
     }
 }

@@ -21,6 +21,7 @@ pub mod counts;
 pub(crate) mod cover;
 pub(crate) mod encode;
 pub mod epo;
+pub mod far;
 pub mod flux;
 pub mod geometry;
 mod hlbvh;

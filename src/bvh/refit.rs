@@ -15,6 +15,7 @@
 //! build again. The twin is [`super::twin::refit`]: the same bytes.
 
 use super::builder;
+use super::far;
 use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout::{NODES_OFFSET, node_slots};
@@ -148,7 +149,7 @@ impl Refit {
     /// The structure must have been built over as many primitives with the same options; it may be compacted. Any other
     /// structure stays as it is. Before, the caller makes input and structure visible to compute shaders. After, it places a
     /// barrier from compute shader writes to whatever reads the structure or writes the scratch memory. Labels: `leaves` and
-    /// `climb`, or `refit` where one workgroup does both.
+    /// `climb`, or `refit` where one workgroup does both; of a top level `far` behind that.
     ///
     /// # Errors
     /// The memory is too small; the input has another number of primitives or geometries than was planned for; a pipeline could
@@ -175,7 +176,7 @@ impl Refit {
         let mut chains = Vec::new();
         // What fills the push constants together must be of one kind.
         let mut kinds: HashMap<(Kernel, [u32; 2]), usize> = HashMap::new();
-        let mut small: Vec<(Kernel, [f32; 2], Vec<arguments::Update>)> = Vec::new();
+        let mut small: Vec<(&Refit, Kernel, Vec<arguments::Update>)> = Vec::new();
         for job in jobs {
             let update = job.update()?;
             let RefitJob { refit, input, .. } = job;
@@ -186,29 +187,33 @@ impl Refit {
                     let groups = update.primitive_count.div_ceil(refit.workgroup * refit.run);
                     let arguments = arguments_of(&[update], costs);
                     let step = |phase, shader| Step::new(phase, refit.kernel(shader, input), &arguments, groups);
-                    chains.push(vec![
-                        step("leaves", &shaders::BVH_REFIT_LEAVES),
-                        step("climb", &shaders::BVH_REFIT_CLIMB),
-                    ]);
+                    let steps = [step("leaves", &shaders::BVH_REFIT_LEAVES), step("climb", &shaders::BVH_REFIT_CLIMB)];
+                    chains.push(steps.into_iter().chain(refit.far_steps(&[update])).collect());
                 }
                 RefitSchedule::Workgroup => {
                     let kernel = refit.kernel(&shaders::BVH_REFIT_WORKGROUP, input);
                     let at = *kinds.entry((kernel.clone(), costs.map(f32::to_bits))).or_insert_with(|| {
-                        small.push((kernel.clone(), costs, Vec::new()));
+                        small.push((*refit, kernel.clone(), Vec::new()));
                         small.len() - 1
                     });
                     small[at].2.push(update);
                 }
             }
         }
-        for (kernel, costs, updates) in &small {
-            chains.extend(
-                updates.chunks(AT_ONCE).map(|pair| {
-                    vec![Step::new("refit", kernel.clone(), &arguments_of(pair, *costs), pair.len() as u32)]
-                }),
-            );
+        for (refit, kernel, updates) in &small {
+            let costs = [refit.costs.c_t, refit.costs.c_i];
+            chains.extend(updates.chunks(AT_ONCE).map(|pair| {
+                let step = Step::new("refit", kernel.clone(), &arguments_of(pair, costs), pair.len() as u32);
+                std::iter::once(step).chain(refit.far_steps(pair)).collect::<Vec<_>>()
+            }));
         }
         Ok(chains)
+    }
+
+    /// Of top levels, what tells again what is far: boxes have moved.
+    fn far_steps(&self, updates: &[arguments::Update]) -> impl Iterator<Item = Step> {
+        let is_top = self.planned.primitives == Primitives::Instances;
+        updates.iter().filter(move |_| is_top).map(|update| far::step(update.structure, true))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Walks a structure on the host and says what is wrong and where.
 
 use super::cover::SplitParts;
+use super::far;
 use super::layout::{Bvh2, Child, Header, InstanceRecord, MAX_DEPTH, Record, node_slots};
 use super::twin::split::around_parts;
 use crate::geometry::Aabb;
@@ -73,6 +74,8 @@ impl<R: Record> Bvh2<R> {
             }
         }
         self.validate_slots(&visited)?;
+        let of_root = self.nodes.get(header.root.index as usize).filter(|_| !header.root.is_leaf());
+        far::validate(header, &self.far, of_root.iter().flat_map(|node| &node.children))?;
         match in_leaf.iter().position(|&there| !there) {
             Some(lost) => invalid(format!("record {lost} is in no leaf")),
             None => parts.check(&self.records),
@@ -166,7 +169,7 @@ fn same_box(child: &Child, around: &Aabb, named_by: &str) -> Result<()> {
     ))
 }
 
-fn invalid(what: String) -> Result<()> {
+pub(crate) fn invalid<T>(what: String) -> Result<T> {
     Err(Error::InvalidStructure(what))
 }
 
@@ -198,7 +201,7 @@ mod tests {
     #[test]
     fn every_broken_rule_is_found_and_named() {
         type Break = fn(&mut Bvh2);
-        let breaks: [(&str, Break); 9] = [
+        let breaks: [(&str, Break); 11] = [
             ("has box", |t| t.nodes[t.header.root.index as usize].children[0].hi[1] += 1.0),
             ("two leaves", |t| first_leaf(t).index = 3),
             ("there are 20 records", |t| first_leaf(t).count = 21),
@@ -207,6 +210,11 @@ mod tests {
             ("the header says 7", |t| t.header.inner_nodes = 7),
             ("18 node slots for 20 records", |t| t.header.node_slots = 18),
             ("20 node slots for 20 records", |t| t.header.node_slots = 20),
+            ("node 0 is near, sides 0b1 far, and 0 boxes", |t| t.header.far_sides = 1),
+            ("is no child of the root", |t| {
+                (t.header.near_node, t.header.far_sides) = (0xFFFF, 1);
+                t.far = [vec![t.header.root.bounds()], vec![Aabb::EMPTY; 5]].concat();
+            }),
             ("slots from there on are unused", |t| {
                 // The root moves behind the slots that its twenty triangles need.
                 t.records.push(Triangle { primitive: 20, ..t.records[0] });

@@ -11,7 +11,7 @@ use hedgerow::accel::{AccelOptions, Instance, REBRAID, Tree, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::layout::Child;
+use hedgerow::bvh::layout::{Child, InstanceRecord};
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::WideNode;
 use hedgerow_lab::random::SplitMix64;
@@ -134,8 +134,7 @@ fn what_is_near_is_opened_before_what_is_far_however_large() {
         let near = side * side * side;
         let opened = |far: &[Instance]| {
             let read = ReadBack::new(&ours, &grid(side, far, Flags::PREFER_FAST_TRACE));
-            let of_near =
-                |record: &&hedgerow::bvh::layout::InstanceRecord| record.structure != 0 && record.instance < near;
+            let of_near = |record: &&InstanceRecord| record.structure != 0 && record.instance < near;
             read.top.records().iter().filter(of_near).count() as u32
         };
         // The budget grows with each far instance by four entries, of which it takes one.
@@ -145,25 +144,33 @@ fn what_is_near_is_opened_before_what_is_far_however_large() {
     }
 }
 
-/// The instances below each child of the root.
-fn below_the_root(read: &ReadBack) -> Vec<BTreeSet<u32>> {
-    let Tree::OfEight(tree) = &read.top else { panic!("a fast trace has nodes of eight") };
+/// What a leaf holds, or the children of a node.
+fn inside(top: &Tree<InstanceRecord>, child: &Child) -> (Vec<InstanceRecord>, Vec<Child>) {
+    let index = child.index as usize;
+    match top {
+        Tree::OfTwo(tree) if child.is_leaf() => (tree.records[index..][..child.count as usize].to_vec(), vec![]),
+        Tree::OfTwo(tree) => (vec![], tree.nodes[index].children.to_vec()),
+        Tree::OfEight(tree) => {
+            let leaf = if child.is_leaf() { Some((child.index, child.count)) } else { tree.nodes[index].long_leaf() };
+            let records = leaf.map(|(first, count)| tree.leaf(first, count).to_vec());
+            let children = || tree.nodes[index].children().into_iter().flatten().collect();
+            records.map_or_else(|| (vec![], children()), |records| (records, vec![]))
+        }
+    }
+}
+
+/// The children of the root, each with the instances below it.
+fn below_the_root(read: &ReadBack) -> Vec<(Child, BTreeSet<u32>)> {
     let below = |child: Child| {
         let (mut instances, mut waiting) = (BTreeSet::new(), vec![child]);
         while let Some(child) = waiting.pop() {
-            let (of_leaf, node) = match child.is_leaf() {
-                true => (Some((child.index, child.count)), None),
-                false => (tree.nodes[child.index as usize].long_leaf(), Some(&tree.nodes[child.index as usize])),
-            };
-            if let Some((first, count)) = of_leaf {
-                let records = &tree.records[tree.places.records(first, count)];
-                instances.extend(records.iter().map(|record| record.instance));
-            }
-            waiting.extend(node.into_iter().flat_map(|node| node.children()).flatten());
+            let (records, children) = inside(&read.top, &child);
+            instances.extend(records.iter().map(|record| record.instance));
+            waiting.extend(children);
         }
-        instances
+        (child, instances)
     };
-    tree.nodes[0].children().into_iter().flatten().map(below).collect()
+    inside(&read.top, &read.top.header().root).1.into_iter().map(below).collect()
 }
 
 /// In cells as large as the way to what is far, all that is near would be one box: it has a node of its own, which costs one node more.
@@ -177,7 +184,7 @@ fn all_that_is_near_is_one_child_of_the_root() {
             let read = ReadBack::new(&ours, &grid(side, far, Flags::PREFER_FAST_TRACE));
             let header = read.top.header();
             assert!(header.inner_nodes <= Form::EightQuantised.nodes_at_most(header.active), "{header:?}");
-            below_the_root(&read)
+            below_the_root(&read).into_iter().map(|(_, below)| below).collect::<Vec<_>>()
         };
         let what = format!("{side}³ and {count} at 2^{e} in {axes}");
         let with_far = root(&far(count, e, axes));
@@ -197,27 +204,29 @@ fn the_header_names_the_node_over_what_is_near_and_the_sides_of_what_is_far() {
         let read = ReadBack::new(&ours, world);
         read.top.validate().expect("valid");
         let header = *read.top.header();
-        let Tree::OfEight(tree) = &read.top else { panic!("a fast trace has nodes of eight") };
-        let of_root = tree.nodes[0].children().into_iter().flatten().zip(below_the_root(&read));
-        let near =
-            of_root.filter(|(child, _)| !child.is_leaf() && child.index == header.near_node).map(|(_, below)| below);
-        (header.far_sides, near.last().filter(|_| header.near_node != 0))
+        let is_near = |child: &Child| header.near_node != 0 && !child.is_leaf() && child.index == header.near_node;
+        let near = below_the_root(&read).into_iter().find(|(child, _)| is_near(child));
+        (header.far_sides, near.map(|(_, below)| below))
     };
-    let with = |far: &[Instance]| grid(4, far, Flags::PREFER_FAST_TRACE);
-    assert_eq!(header_of(&with(&[])), (0, None));
-    let all_near = Some((0..64).collect());
-    for (count, axes, e, sides) in [(1, 1, 14, 0b10), (1, 3, 60, 0b10), (20, 1, 60, 0b11), (8, 3, 9, 0b11)] {
-        assert_eq!(header_of(&with(&far(count, e, axes))), (sides, all_near.clone()), "{count} at 2^{e} in {axes}");
+    // In nodes of eight, and of two.
+    for flags in [Flags::PREFER_FAST_TRACE, Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE | Flags::ALLOW_UPDATE] {
+        let with = |far: &[Instance]| grid(4, far, flags);
+        assert_eq!(header_of(&with(&[])), (0, None), "{flags:?}");
+        let all_near = Some((0..64).collect());
+        for (count, axes, e, sides) in [(1, 1, 14, 0b10), (1, 3, 60, 0b10), (20, 1, 60, 0b11), (8, 3, 9, 0b11)] {
+            let what = format!("{count} at 2^{e} in {axes}, {flags:?}");
+            assert_eq!(header_of(&with(&far(count, e, axes))), (sides, all_near.clone()), "{what}");
+        }
+        // Along y and z, and what is large but reaches into none of the others.
+        let beside =
+            [[3.0, 4000.0, 1.0], [0.0, -4000.0, 2.0], [1.0, 2.0, -9000.0]].map(|to| Instance::new(1, scaled(2.0, to)));
+        assert_eq!(header_of(&with(&beside)), (0b01_1100, all_near), "{flags:?}");
+        // What is far, and one triangle that reaches through everything: a ray may meet that anywhere.
+        let mut world = with(&far(1, 14, 1));
+        world.parts.push(part(vec![[[-1.0; 3], [1.0; 3], [1.0, -1.0, 0.0]]]));
+        world.instances.push(Instance::new(3, scaled(1000.0, [0.0; 3])));
+        assert_eq!(header_of(&world), (0, None), "{flags:?}");
     }
-    // Along y and z, and what is large but reaches into none of the others.
-    let beside =
-        [[3.0, 4000.0, 1.0], [0.0, -4000.0, 2.0], [1.0, 2.0, -9000.0]].map(|to| Instance::new(1, scaled(2.0, to)));
-    assert_eq!(header_of(&with(&beside)), (0b01_1100, all_near));
-    // What is far, and one triangle that reaches through everything: a ray may meet that anywhere.
-    let mut world = with(&far(1, 14, 1));
-    world.parts.push(part(vec![[[-1.0; 3], [1.0; 3], [1.0, -1.0, 0.0]]]));
-    world.instances.push(Instance::new(3, scaled(1000.0, [0.0; 3])));
-    assert_eq!(header_of(&world), (0, None));
 }
 
 /// From what is near to what is near, to what is far and past it, up to limits before and behind.
@@ -225,14 +234,15 @@ fn the_header_names_the_node_over_what_is_near_and_the_sides_of_what_is_far() {
 fn rays_meet_what_is_near_and_what_is_far_as_by_brute_force() {
     let ours = Ours::on(device());
     let mut random = SplitMix64::new(5);
-    for axes in [1, 3] {
+    let flags_of_forms = [Flags::PREFER_FAST_TRACE, Flags::PREFER_FAST_BUILD];
+    for (axes, flags_of_form) in [1, 3].into_iter().flat_map(|axes| flags_of_forms.map(|form| (axes, form))) {
         // Beside each other, so that a ray tells which it meets.
         let beside = |(i, far): (usize, &Instance)| {
             let [x, y, z] = far.transform.map(|row| row[3]);
             Instance::new(2, scaled(6.0, [x, y + 20.0 * i as f32, z]))
         };
         let far: Vec<Instance> = far(6, 7, axes).iter().enumerate().map(beside).collect();
-        let world = grid(4, &far, Flags::PREFER_FAST_TRACE);
+        let world = grid(4, &far, flags_of_form);
         assert_ne!(ReadBack::new(&ours, &world).top.header().near_node, 0);
         let ray = |i: usize| {
             let origin: [f32; 3] = std::array::from_fn(|_| 1.5 + 2.5 * random.signed());
@@ -246,7 +256,7 @@ fn rays_meet_what_is_near_and_what_is_far_as_by_brute_force() {
             ProbeRay { flags: which, decision: CONFIRM, t_max, ..ProbeRay::new(origin, direction) }
         };
         let rays: Vec<ProbeRay> = (0..600).map(ray).collect();
-        let hits = assert_agrees(&ours, &format!("far in {axes} axes"), &world, &rays);
+        let hits = assert_agrees(&ours, &format!("far in {axes} axes, {flags_of_form:?}"), &world, &rays);
         assert!(hits > 150, "{hits} hits are no test");
     }
 }

@@ -1,13 +1,15 @@
 //! Updates: structures whose primitives have moved, in place and from another, through ours and the driver's.
 
 use crate::common::agree::assert_reports;
-use crate::common::backends::{Backend, Built, backends};
+use crate::common::backends::{Backend, Built, Ours, backends};
 use crate::common::device;
+use crate::common::mixture::scaled;
 use crate::common::probe::ProbeRay;
 use crate::common::shapes::{boxes, soup};
 use crate::common::world::{Part, World};
-use hedgerow::accel::Instance;
+use hedgerow::accel::{Instance, Tree};
 use hedgerow::ash::vk;
+use hedgerow::bvh::layout::InstanceRecord;
 use hedgerow_lab::random::SplitMix64;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::BuildAccelerationStructureModeKHR as Mode;
@@ -197,5 +199,58 @@ fn top_levels_follow_their_instances() {
             backend.destroy(built.top.structure);
             built.parts.iter().for_each(|part| backend.destroy(part.structure));
         }
+    }
+}
+
+/// Rays begin at what is near where the header tells what is far: after an update, too, whether something came from there or went.
+#[test]
+fn instances_that_come_from_far_and_go_there_are_met_where_they_are() {
+    let ours = Ours::on(device());
+    let world = |last: f32| {
+        let near = (0..27).map(|i| scaled(0.8, [i % 3, i / 3 % 3, i / 9].map(|k| k as f32 - 1.0)));
+        let instances = near.chain([scaled(30.0, [last, 0.0, 0.0])]).map(|to_world| Instance::new(1, to_world));
+        let flags = Flags::ALLOW_UPDATE | Flags::PREFER_FAST_TRACE;
+        World {
+            flags,
+            ..World::new(vec![Part::Triangles(vec![(soup(12, 0.3, 1), GeometryFlags::OPAQUE)])], instances.collect())
+        }
+    };
+    let told = |built: &Built| {
+        let read = Tree::<InstanceRecord>::from_bytes(&built.memory.read::<u8>(built.bytes as usize)).expect("built");
+        read.validate().expect("valid");
+        (read.header().near_node != 0, read.header().far_sides)
+    };
+    let far = [(true, 0b01), (true, 0b10)];
+    let none = (false, 0);
+    // Where nothing was far there may be no room to tell of it.
+    for (from, to, before, after) in [
+        (4000.0, 3.0, far[1], none),
+        (4000.0, 9000.0, far[1], far[1]),
+        (-4000.0, 700.0, far[0], far[1]),
+        (3.0, 4000.0, none, none),
+    ] {
+        let what = format!("from {from} to {to}");
+        let moved = world(to);
+        let built = world(from).build(&ours);
+        assert_eq!(told(&built.top), before, "{what}");
+        built.instances.write(&moved.placed(&ours, &built.parts));
+        let geometries = [built.geometry];
+        let asked = info(vk::AccelerationStructureTypeKHR::TOP_LEVEL, &geometries);
+        update(&ours, asked, &[Range::default().primitive_count(28)], &built.top, &built.top);
+        assert_eq!(told(&built.top), after, "{what}");
+        let mut random = SplitMix64::new(7);
+        let ray = |i: usize| {
+            let origin = random.around(2.0);
+            let (around, along) = [(1.2, 0.0), (9.0, to)][i % 2];
+            let [x, y, z] = random.around(around);
+            let target = [x + along, y, z];
+            ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]))
+        };
+        let rays: Vec<ProbeRay> = (0..300).map(ray).collect();
+        let reports = ours.probe(built.top.structure, &rays);
+        let hits = assert_reports(&what, &moved, &rays, &reports);
+        assert!(hits > 60, "{what}: {hits} hits are no test");
+        ours.destroy(built.top.structure);
+        built.parts.iter().for_each(|part| ours.destroy(part.structure));
     }
 }

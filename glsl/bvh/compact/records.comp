@@ -1,5 +1,5 @@
 #version 460
-// The records of the tree and the table of geometries: see bvh/compact.glsl for the contract.
+// The records of the tree and what lies behind them: see bvh/compact.glsl for the contract.
 #include "bvh/compact.glsl"
 
 void main() {
@@ -12,5 +12,7 @@ void main() {
     Words given = Words(geometry_table_of(uvec2(source), from));
     Words table = Words(geometry_table_of(uvec2(target), to));
     uint words = to.geometry_count > 1 ? 2 * to.geometry_count : 0;
+    // Or the boxes of what is far, in a top level.
+    if (to.near_node != 0) words = FAR_SIDES * FAR_BOX_BYTES / 4;
     for (uint k = 0, i = grid_item(0); i < words; i = grid_item(++k)) table.word[i] = given.word[i];
 }

@@ -47,7 +47,11 @@ void make(uint link, Move m) {
 }
 
 void make_moves() {
-    if (grid_item(0) == 0u) structure.header.child_order = 0u;
+    if (grid_item(0) == 0u) {
+        structure.header.child_order = 0u;
+        structure.header.near_node = 0u;
+        structure.header.far_sides = 0u;
+    }
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
         Move m = moves.move[i];
         if (m.to != NONE) make(link_of(i), m);

@@ -90,7 +90,7 @@ uint put_near_and_far() {
         uint name = take_next() & NAME;
         Child other = child_named(name);
         waiting--;
-        if (side_of(near, other) != ON_NO_SIDE) {
+        if (side_of(near, other, source.header.area_scale) != ON_NO_SIDE) {
             put_child(count, name, other);
             count++;
         } else if (is_inner(other) && count + waiting + 2 <= WIDTH) {

@@ -1,28 +1,9 @@
-// What is far from the rest of a top level: a part of the steps `open` and `nodes` of bvh/wide/collapse.glsl. src/bvh/wide/far.rs says what it is
-// for, src/bvh/twin/wide/far.rs is the twin.
+// What is far from the rest of a top level in nodes of eight: a part of the steps `open` and `nodes` of bvh/wide/collapse.glsl.
+// src/bvh/far.rs says what it is for, src/bvh/twin/far.rs is the twin.
 #ifndef HEDGEROW_BVH_WIDE_FAR
 #define HEDGEROW_BVH_WIDE_FAR
 #include "bvh/wide/collapse.glsl"
-
-// src/bvh/wide/far.rs
-const float FAR_BY = 0.5;
-
-const uint ON_NO_SIDE = FAR_SIDES;
-
-// The side of what is near to which another child lies by more than FAR_BY of its longest edges, the first one.
-uint side_of(Child near, Child other) {
-    float scale = source.header.area_scale;
-    vec3 edges = scaled_edges(Box(near.lo, near.hi), scale);
-    float least = max(FAR_BY * max(max(edges.x, edges.y), edges.z), SHORTEST);
-    precise vec3 below = near.lo * scale - other.hi * scale;
-    precise vec3 above = other.lo * scale - near.hi * scale;
-    uint side = ON_NO_SIDE;
-    for (uint axis = 3; axis-- > 0;) {
-        side = above[axis] > least ? 2 * axis + 1 : side;
-        side = below[axis] > least ? 2 * axis : side;
-    }
-    return side;
-}
+#include "bvh/far.glsl"
 
 // What names the first child of a top level's root, if that is a node: what is near, where something is far. Otherwise NO_CHILD.
 uint name_of_near() {
@@ -39,8 +20,7 @@ void tell_far(uint next_node) {
     if (first == NO_CHILD) return;
     Child near = child_named(first);
     FarBoxes boxes = FarBoxes(far_boxes_of(target, Structure(target).header));
-    FarBox nothing = FarBox(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-    for (uint side = 0; side < FAR_SIDES; ++side) boxes.box[side] = nothing;
+    for (uint side = 0; side < FAR_SIDES; ++side) boxes.box[side] = far_box_of_nothing();
     uint near_node = 0, sides = 0;
     NextSlots of_root = slots_of(0);
     for (uint s = 0; s < 8; ++s) {
@@ -50,7 +30,7 @@ void tell_far(uint next_node) {
         if (in_slot == first) {
             near_node = next_node;
         } else {
-            uint side = side_of(near, child);
+            uint side = side_of(near, child, source.header.area_scale);
             if (side == ON_NO_SIDE) return;
             FarBox b = boxes.box[side];
             boxes.box[side] = FarBox(min(b.lo, child.lo), max(b.hi, child.hi));

@@ -54,6 +54,9 @@ void write_header(bool there_is) {
     if (!is_binary(header)) header = header_of_wrong_version();
     header = compacted(header);
     uint nodes = there_is ? 1 + nodes_before_block(block_count()) : 0;
+    // What is far is told of this tree.
+    header.near_node = 0;
+    header.far_sides = 0;
     header.kind = wide_kind(header.kind, WIDTH, QUANTISED);
     header.root.index = 0;
     header.root.count = 0;

@@ -48,7 +48,7 @@ pub(super) fn collapse<B: Boxed>(tree: &mut Topology, records: &[B], collapse: &
 /// The tree itself.
 pub(super) fn layout<R: Record>(input: &Input, tree: &Topology, collapsed: &Collapsed, records: Vec<R>) -> Bvh2<R> {
     let (header, nodes) = layout_over(input.header::<R>(), input, tree, collapsed, &records);
-    Bvh2 { header, nodes, records, geometries: Vec::new() }
+    Bvh2 { header, nodes, records, geometries: Vec::new(), far: Vec::new() }
 }
 
 /// The tree over parts of primitives: its leaves have the boxes of `parts`, which are as many as the records.
@@ -60,7 +60,7 @@ pub(super) fn layout_parts<R: Record>(
     records: Vec<R>,
 ) -> Bvh2<R> {
     let (header, nodes) = layout_over(input.header::<R>(), input, tree, collapsed, parts);
-    Bvh2 { header, nodes, records, geometries: Vec::new() }
+    Bvh2 { header, nodes, records, geometries: Vec::new(), far: Vec::new() }
 }
 
 fn layout_over<B: Boxed>(

@@ -33,6 +33,7 @@ impl<R: Record> Bvh2<R> {
             self.header.child_order = 1;
             let ordering = Ordering { order, costs: *costs, scale: self.header.area_scale };
             ordering.subtree(&mut self, counts, root.index);
+            return self.with_nothing_far();
         }
         self
     }

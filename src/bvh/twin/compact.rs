@@ -12,12 +12,15 @@ impl Header {
             header.root = Child { lo: Aabb::EMPTY.lo, index: 0, hi: Aabb::EMPTY.hi, count: 0 };
             header.active = 0;
             header.inner_nodes = 0;
+            (header.near_node, header.far_sides) = (0, 0);
         }
         header.primitive_count = header.active;
         header.node_slots = header.inner_nodes.max(1);
         if !header.root.is_leaf() {
             header.root.index = 0;
         }
+        // What is near is the root's left child.
+        header.near_node = header.near_node.min(1);
         header
     }
 }
@@ -33,7 +36,8 @@ impl<R: Record> Bvh2<R> {
         }
         nodes.resize(header.node_slots as usize, Node::UNUSED);
         let records = self.records[..header.active as usize].to_vec();
-        Bvh2 { header, nodes, records, geometries: self.geometries.clone() }
+        let far = if header.near_node == 0 { Vec::new() } else { self.far.clone() };
+        Bvh2 { header, nodes, records, geometries: self.geometries.clone(), far }
     }
 
     /// Appends the subtree; what names it now.

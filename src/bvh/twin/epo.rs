@@ -171,7 +171,7 @@ mod tests {
             node_slots: nodes.len() as u32,
             ..Header::zeroed()
         };
-        Bvh2 { header, nodes, records: records.iter().map(record).collect(), geometries: Vec::new() }
+        Bvh2 { header, nodes, records: records.iter().map(record).collect(), geometries: Vec::new(), far: Vec::new() }
     }
 
     #[test]

@@ -116,7 +116,7 @@ pub fn build_boxes<R: Record>(
         }
     };
     header.inner_nodes = tree.nodes.iter().filter(|node| node.is_used()).count() as u32;
-    Bvh2 { header, nodes: tree.nodes, records: tree.records, geometries: Vec::new() }
+    Bvh2 { header, nodes: tree.nodes, records: tree.records, geometries: Vec::new(), far: Vec::new() }
 }
 
 impl<R: Record> Bvh2<R> {

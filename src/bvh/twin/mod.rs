@@ -6,6 +6,7 @@ mod clusters;
 mod collapse;
 mod compact;
 pub mod epo;
+mod far;
 pub mod geometry;
 pub mod hlbvh;
 pub mod hploc;

@@ -48,6 +48,9 @@ pub fn refit_boxes<R: Record>(
     let mut root = tree.header.root;
     tree.header.cost = subtree(tree, &leaf_boxes, costs, &mut root);
     tree.header.root = root;
+    if tree.header.near_node != 0 {
+        *tree = tree.clone().with_far_told();
+    }
 }
 
 /// Gives `child` and all below it their boxes. Returns the cost.

@@ -120,6 +120,7 @@ impl<R: Record> Bvh2<R> {
         }
         if rounds > 0 {
             work.tree.header.child_order = 0;
+            return work.tree.with_nothing_far();
         }
         work.tree
     }

@@ -1,9 +1,9 @@
 //! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
 
 mod costs;
-mod far;
 
 use self::costs::{Choice, choices_of};
+use super::far;
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::sah::half_area_of_edges;
@@ -48,6 +48,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             assert!(counts.is_empty() || counts.len() >= 2 * tree.nodes.len(), "two counts a node slot");
         }
         let mut header = tree.header.compacted();
+        (header.near_node, header.far_sides) = (0, 0);
         header.kind = Self::KIND;
         (header.root.index, header.root.count) = (0, 0);
         (header.node_slots, header.inner_nodes) = (1, 0);
@@ -92,8 +93,8 @@ impl<N: WideNode, R: Record> Wide<N, R> {
                 }
                 (child.index, child.count) = (index, 0);
             }
-            if node.place.is_none() {
-                far = far::tell_far::<N, R>(tree, &node.children, &children, &mut header);
+            if node.place.is_none() && N::FORM.is_quantised() {
+                far = far::tell_far(tree, &node.children, &children, &mut header);
             }
             let index = node.place.map_or(0, |(parent, rank)| first_children[&parent] + rank);
             nodes[index as usize] = N::of(&children);
@@ -201,7 +202,7 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
         let mut next_level = Vec::new();
         for (root, place) in this_level {
             let is_closed = |child: &Child| level == 0 && N::FORM.is_quantised() && is_closed(tree, child);
-            let apart = if level == 0 { far::root_links::<N, R>(tree) } else { None };
+            let apart = if level == 0 && N::FORM.is_quantised() { far::root_links(tree) } else { None };
             let children = open(tree, &choices, (&root, level, apart), is_closed, width, counts.ordered_by);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() && tree.header.child_order == 0 {

@@ -1,7 +1,8 @@
 //! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`crate::bvh::twin::wide`] is the twin.
 
-use super::{Form, far, pairs};
+use super::{Form, pairs};
 use crate::bvh::counts::LinkCount;
+use crate::bvh::far;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{NODES_OFFSET, node_slots};
 use crate::gpu::arguments;

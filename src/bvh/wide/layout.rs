@@ -8,7 +8,7 @@
 //! | nodes × `node_slots` | [`Form::node_bytes`] each | [`NODES_OFFSET`] |
 //! | [`Record`] × `primitive_count` | 40, 28 or 128 each; of quantised trees two triangles may be one record of 56 ([`super::pairs`]) | behind the nodes |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
-//! | [`Aabb`] × 6, of a quantised top level that has something far ([`super::far`]) | 24 each | behind the records |
+//! | [`Aabb`] × 6, of a quantised top level that has something far ([`crate::bvh::far`]) | 24 each | behind the records |
 //!
 //! The header is that of a `Bvh2` with another `kind`: [`Form::kind`]. The root is node 0, always, even if the whole tree is a
 //! leaf: then it has one child. `node_slots` are the nodes that there are, at least one, `primitive_count` the records in leaves.
@@ -17,8 +17,9 @@
 //! Nodes of floats hold [`Child`]ren as those of a `Bvh2` do, the first ones used, the others [`Child::UNUSED`]; records lie in
 //! the order of the binary tree. [`super::quantised`] describes quantised ones.
 
+use super::Form;
 use super::pairs::{self, Places, SAVED_BY_PAIR};
-use super::{Form, far};
+use crate::bvh::far;
 use crate::bvh::layout::{self, Child, GeometryEntry, Header, NODES_OFFSET, Record, Triangle, header_of};
 use crate::geometry::Aabb;
 use crate::{Error, Result};

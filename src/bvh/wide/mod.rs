@@ -10,14 +10,12 @@
 //! Where the children of the source have an order ([`super::child_order`]), those of a wide node lie in their slots as rays shall look
 //! into them that end at any hit, and the header says so, too.
 //!
-//! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes, [`pairs`] those of triangles that share an edge, [`far`] those of
-//!   what is far from the rest of a top level;
+//! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes, [`pairs`] those of triangles that share an edge;
 //! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
 //! - [`validate`] walks a wide tree, [`quality`] says what it costs;
 //! - [`crate::trace::wide`] traces it.
 
 pub mod device;
-pub mod far;
 pub mod layout;
 pub mod pairs;
 pub mod quality;

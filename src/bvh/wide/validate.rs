@@ -1,13 +1,13 @@
 //! Walks a wide tree on the host and says what is wrong and where.
 
-use super::far;
 use super::layout::{Wide, WideNode, leaf_max};
+use crate::Result;
 use crate::bvh::cover::SplitParts;
-use crate::bvh::layout::{Header, InstanceRecord, Record};
+use crate::bvh::far;
+use crate::bvh::layout::{InstanceRecord, Record};
 use crate::bvh::twin::split::around_parts;
-use crate::bvh::validate::validate_split_primitives;
+use crate::bvh::validate::{invalid, validate_split_primitives};
 use crate::geometry::Aabb;
-use crate::{Error, Result};
 
 impl<N: WideNode, R: Record> Wide<N, R> {
     /// Checks every rule of the layout: indices in range, no cycle, every record in exactly one leaf and every node named by
@@ -18,7 +18,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
     /// them as in [`Bvh2::validate`](crate::bvh::layout::Bvh2::validate).
     ///
     /// # Errors
-    /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
+    /// [`Error::InvalidStructure`](crate::Error::InvalidStructure) names the first node that breaks a rule, and the rule.
     pub fn validate(&self) -> Result<()> {
         self.validate_counts()?;
         if self.header.active == 0 {
@@ -38,7 +38,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if let Some(node) = visited.iter().position(|&visited| !visited) {
             return invalid(format!("node {node} is named by none"));
         }
-        self.validate_far()?;
+        far::validate(&self.header, &self.far, self.nodes[0].children().iter().flatten())?;
         match in_leaf.iter().position(|&named| !named) {
             Some(record) => invalid(format!("record {record} is in no leaf")),
             None => parts.check(&self.records),
@@ -78,26 +78,6 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             return invalid(format!("{} pairs of records, and {pairs} are there", header.pairs));
         }
         self.validate_primitives()
-    }
-
-    /// Where something is far, the root names the node over what is not, and the sides that the header names, and no others, have a box.
-    fn validate_far(&self) -> Result<()> {
-        let Header { near_node, far_sides, .. } = self.header;
-        let there = if near_node == 0 { 0 } else { far::SIDES };
-        let sides = far::sides_of(&self.far);
-        if self.far.len() != there || sides != far_sides || (sides == 0) != (near_node == 0) {
-            let boxes = self.far.len();
-            return invalid(format!(
-                "node {near_node} is near, sides {far_sides:#b} far, and {boxes} boxes on {sides:#b}"
-            ));
-        }
-        let of_root = self.nodes[0].children();
-        let is_named = of_root.iter().flatten().any(|child| !child.is_leaf() && child.index == near_node);
-        match self.far.iter().find(|b| **b != Aabb::EMPTY && !self.header.root.bounds().contains(b)) {
-            _ if near_node != 0 && !is_named => invalid(format!("the near node {near_node} is no child of the root")),
-            Some(b) => invalid(format!("what is far has box {b:?}, outside of the root's")),
-            None => Ok(()),
-        }
     }
 
     /// The primitive order names every primitive once; of a top level, an instance may have several entries.
@@ -208,10 +188,6 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             around => Ok(around),
         }
     }
-}
-
-fn invalid<T>(what: String) -> Result<T> {
-    Err(Error::InvalidStructure(what))
 }
 
 #[cfg(test)]

@@ -7,13 +7,15 @@ use hedgerow::bvh::layout::{Bvh2, Child, Header, Record};
 use hedgerow::bvh::wide::layout::{Wide8q, WideNode};
 use hedgerow::geometry::Aabb;
 
-/// (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(`part`), of boxes clipped to `part`; `None` where that has no area.
+/// (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(`part`), of boxes clipped to `part`; `None` where that has no area. Where something is
+/// far, rays begin at the node over what is near, wherever they go, and those that meet something far at the root
+/// ([`hedgerow::bvh::far`]).
 pub fn cost<R: Record>(tree: &Bvh2<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
-    cost_below(&tree.header, |inner| tree.nodes[inner.index as usize].children.to_vec(), part, [c_t, c_i])
+    let below = |inner: &Child| tree.nodes[inner.index as usize].children.to_vec();
+    cost_from_near((&tree.header, &tree.far), below, part, [c_t, c_i])
 }
 
-/// The same of a tree in nodes of eight, of a step at one of them, by the boxes that rays see. Where something is far, rays begin at the node
-/// over what is near, wherever they go, and those that meet something far at the root ([`hedgerow::bvh::wide::far`]).
+/// The same of a tree in nodes of eight, of a step at one of them, by the boxes that rays see.
 pub fn cost_of_eight<R: Record>(tree: &Wide8q<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
     let below = |inner: &Child| {
         let node = &tree.nodes[inner.index as usize];
@@ -22,36 +24,53 @@ pub fn cost_of_eight<R: Record>(tree: &Wide8q<R>, part: &Aabb, c_t: f64, c_i: f6
             None => node.children().into_iter().flatten().collect(),
         }
     };
-    let cost = cost_below(&tree.header, below, part, [c_t, c_i])?;
-    let near = tree.nodes[0].children().into_iter().flatten().find(|child| child.index == tree.header.near_node);
-    let near = near.filter(|_| tree.header.near_node != 0);
-    Some(near.map_or(cost, |near| {
-        let whole = clipped_half_area(part, part);
-        let part_of = |b: &Aabb| clipped_half_area(b, part) / whole;
-        let far = tree.far.iter().map(part_of).sum::<f64>().min(1.0);
-        cost + c_t * (far - part_of(&tree.header.root.bounds()) + 1.0 - part_of(&near.bounds()))
-    }))
+    cost_from_near((&tree.header, &tree.far), below, part, [c_t, c_i])
 }
 
-/// The same of any tree, with what is below an inner child.
-fn cost_below(header: &Header, children: impl Fn(&Child) -> Vec<Child>, part: &Aabb, costs: [f64; 2]) -> Option<f64> {
-    let [c_t, c_i] = costs;
+/// The same of any tree with its boxes of what is far, with what is below an inner child.
+fn cost_from_near(
+    (header, far): (&Header, &[Aabb]),
+    children: impl Fn(&Child) -> Vec<Child>,
+    part: &Aabb,
+    costs: [f64; 2],
+) -> Option<f64> {
     let whole = clipped_half_area(part, part);
     if whole.is_nan() || whole <= 0.0 {
         return None;
     }
+    let share = |b: &Aabb| clipped_half_area(b, part) / whole;
+    let [c_t, _] = costs;
+    if header.active == 0 || header.near_node == 0 {
+        let root = if header.active == 0 { vec![] } else { vec![header.root] };
+        return Some(cost_below(root, &children, share, costs));
+    }
+    let is_near = |child: &Child| !child.is_leaf() && child.index == header.near_node;
+    let (near, others): (Vec<Child>, Vec<Child>) = children(&header.root).into_iter().partition(is_near);
+    // As many rays as meet something far.
+    let far = far.iter().map(share).sum::<f64>().min(1.0);
+    let at_most_far = |b: &Aabb| share(b).min(far);
+    let of_near = c_t + cost_below(near.iter().flat_map(&children).collect(), &children, share, costs);
+    Some(c_t * far + of_near + cost_below(others, &children, at_most_far, costs))
+}
+
+/// Of these subtrees, of which rays enter a box by its share.
+fn cost_below(
+    mut below: Vec<Child>,
+    children: impl Fn(&Child) -> Vec<Child>,
+    share: impl Fn(&Aabb) -> f64,
+    [c_t, c_i]: [f64; 2],
+) -> f64 {
     let mut cost = 0.0;
-    let mut below = if header.active == 0 { vec![] } else { vec![header.root] };
     while let Some(child) = below.pop() {
-        let area = clipped_half_area(&child.bounds(), part);
+        let share = share(&child.bounds());
         if child.is_leaf() {
-            cost += c_i * area * f64::from(child.count);
+            cost += c_i * share * f64::from(child.count);
         } else {
-            cost += c_t * area;
+            cost += c_t * share;
             below.extend(children(&child));
         }
     }
-    Some(cost / whole)
+    cost
 }
 
 /// Half the surface area of what `b` and `part` share; 0 where they are apart.
@@ -126,6 +145,26 @@ mod tests {
         let met = (2.0 * 5.0 + 5.0 * 0.5 + 0.5 * 2.0) / (6.0 * 5.0 + 5.0 * 1.0 + 1.0 * 6.0);
         let cost = cost_of_eight(&wide, &part, 3.0, 2.0).expect("an area");
         assert!((from_the_root - 3.0 + 3.0 * met - cost).abs() < 1e-9, "{from_the_root} {cost}");
+    }
+
+    /// The node over what is far on two sides is around the part, too, but no ray comes there that meets none of it.
+    #[test]
+    fn in_nodes_of_two_rays_that_begin_near_meet_no_node_over_what_is_far() {
+        let part = Aabb { lo: [0.0; 3], hi: [4.0, 1.0, 1.0] };
+        let at = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]];
+        let robust = "emc64var+apart".parse().expect("codes");
+        let boxes: Vec<[[f32; 3]; 2]> = (0..4).map(|i| at(i as f32)).chain([-1e6, 1e6].map(at)).collect();
+        let positions: Vec<[f32; 3]> = boxes.iter().flat_map(|&[lo, hi]| [lo, hi, [hi[0], lo[1], hi[2]]]).collect();
+        let triangles: Vec<[u32; 3]> = (0..6).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut tree = lbvh::build(&positions, &triangles, robust, Collapse::OFF);
+        let [near, others] = tree.nodes[tree.header.root.index as usize].children;
+        assert!(!others.is_leaf() && near.bounds() == part, "{near:?} {others:?}");
+        let from_the_root = cost(&tree, &part, 3.0, 2.0).expect("an area");
+        (tree.header.near_node, tree.header.far_sides) = (near.index, 0b11);
+        tree.far = [[-1e6], [1e6]].concat().into_iter().map(at).map(|[lo, hi]| Aabb { lo, hi }).collect();
+        tree.far.resize(6, Aabb::EMPTY);
+        let cost = cost(&tree, &part, 3.0, 2.0).expect("an area");
+        assert!((from_the_root - 6.0 - cost).abs() < 1e-9, "{from_the_root} {cost}");
     }
 
     #[test]

@@ -234,7 +234,7 @@ fn converted<'m, const SPLIT: bool>(built: &BvhResult<'_, Triangles<'m, SPLIT>>,
     header.active = records.len() as u32;
     header.primitive_count = header.active;
     header.node_slots = nodes.len() as u32;
-    Bvh2 { header, nodes, records, geometries: Vec::new() }
+    Bvh2 { header, nodes, records, geometries: Vec::new(), far: Vec::new() }
 }
 
 impl<'id, const SPLIT: bool> Conversion<'_, 'id, '_, SPLIT> {

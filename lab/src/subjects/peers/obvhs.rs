@@ -128,7 +128,7 @@ fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
     };
     let mut header = Header { magic: MAGIC, kind: OurTriangle::KIND, ..Header::zeroed() };
     let Some(root) = tree.nodes.first() else {
-        return Bvh2 { header, nodes: Vec::new(), records: Vec::new(), geometries: Vec::new() };
+        return Bvh2 { header, nodes: Vec::new(), records: Vec::new(), geometries: Vec::new(), far: Vec::new() };
     };
     header.root = child(root, 0);
     header.active = tree.primitive_indices.len() as u32;
@@ -159,7 +159,7 @@ fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
         OurTriangle { v0, v1, v2, primitive }
     };
     let records = tree.primitive_indices.iter().map(record).collect();
-    Bvh2 { header, nodes, records, geometries: Vec::new() }
+    Bvh2 { header, nodes, records, geometries: Vec::new(), far: Vec::new() }
 }
 
 impl Subject for Obvhs {
