@@ -17,7 +17,7 @@
 // What is written in a branch or lives through the loop is a word, 1 or 0, and no bool. lavapipe keeps bools in bytes: for each of them that a branch
 // may write, the mask of the lanes is packed, and a condition is unpacked. Queries of two levels are 1.03 times as fast so, in turn 1.06.
 //
-// Rays that meet nothing far of a top level begin at the node over what is near (src/bvh/wide/far.rs).
+// Rays that meet nothing far of a top level begin at the node over what is near (src/bvh/far.rs).
 //
 // Structures are of nodes of two or of nodes of eight (bvh/wide.glsl), which are walked as trace/walk_quantised.glsl does, in either level
 // beside each other. A shader may define HEDGEROW_FORMS, a constant or specialisation constant: which of them there are,
