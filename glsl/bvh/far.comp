@@ -10,7 +10,7 @@
 
 layout(push_constant, scalar) uniform FarArguments {
     Structure structure;
-    uint is_update;   // of what has no boxes yet, and so maybe no room for them
+    uint is_update;   // then what has no boxes yet gets none: there may be no room for them
 };
 
 // src/bvh/far.rs

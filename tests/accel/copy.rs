@@ -11,7 +11,7 @@ use hedgerow::accel::{self, Property, Tree};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::builder::{BuildOptions, Builder};
-use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
 use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Header, InstanceRecord, Record, status};
 use hedgerow::bvh::sah::Collapse;
@@ -85,11 +85,22 @@ fn boxes(count: usize, collapse: Collapse) -> Bvh2<BoxRecord> {
 
 /// Instances of structures at made-up addresses; every fourth is left out.
 fn instances(count: u32) -> Bvh2<InstanceRecord> {
-    let boxes: Vec<Result<Aabb, u32>> = soup(count as usize, 0.1, 5)
-        .iter()
-        .enumerate()
-        .map(|(i, c)| if i % 4 == 1 { Err(status::BAD_INSTANCE) } else { Ok(Aabb::around(c)) })
-        .collect();
+    instances_in(&soup_boxes(count), Code::Mc30.full())
+}
+
+fn instances_and_one_far(count: u32) -> Bvh2<InstanceRecord> {
+    let far = Ok(Aabb { lo: [1e6; 3], hi: [2e6; 3] });
+    let boxes: Vec<Result<Aabb, u32>> = soup_boxes(count).into_iter().chain([far]).collect();
+    instances_in(&boxes, "emc64var+apart".parse().expect("codes")).with_far_told()
+}
+
+fn soup_boxes(count: u32) -> Vec<Result<Aabb, u32>> {
+    let soup = soup(count as usize, 0.1, 5);
+    let boxes = soup.iter().map(|corners| Aabb::around(corners)).enumerate();
+    boxes.map(|(i, b)| if i % 4 == 1 { Err(status::BAD_INSTANCE) } else { Ok(b) }).collect()
+}
+
+fn instances_in(boxes: &[Result<Aabb, u32>], codes: Codes) -> Bvh2<InstanceRecord> {
     let record = |instance: u32| InstanceRecord {
         structure: if instance % 4 == 1 { 0 } else { 0x1_0000_0000 * u64::from(instance) + 256 },
         instance,
@@ -97,7 +108,7 @@ fn instances(count: u32) -> Bvh2<InstanceRecord> {
         to_world: [[instance as f32; 4]; 3],
         ..bytemuck::Zeroable::zeroed()
     };
-    lbvh::build_boxes(&boxes, record, Code::Mc30.full(), Collapse::OFF)
+    lbvh::build_boxes(boxes, record, codes, Collapse::OFF)
 }
 
 fn cases() -> Vec<Case> {
@@ -122,6 +133,10 @@ fn cases() -> Vec<Case> {
         cases.push(Case::wide(&name, &tree));
         cases.push(Case::new(name, &tree));
     }
+    let (name, tree) = ("500 instances and one far away", instances_and_one_far(500));
+    assert!(tree.header.near_node != 0 && Wide8q::of(&tree).header.near_node != 0);
+    cases.push(Case::wide(name, &tree));
+    cases.push(Case::new(name, &tree));
     // None of the triangles is left.
     let nowhere: Corners = vec![[[f32::INFINITY; 3]; 3]; 9];
     cases.push(Case::new("all inactive", &tree_with(&nowhere, Collapse::SAH)));

@@ -6,6 +6,7 @@ use crate::common::{corpus, device, with_tuning};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::far;
 use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Record};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
@@ -124,6 +125,17 @@ fn builds_have_the_order_of_the_host() {
             }
         }
     }
+}
+
+/// What is near would be another child of the root then.
+#[test]
+fn an_order_leaves_what_is_far_untold() {
+    let mut tree = tree_of(&soup(300, 0.1, 4));
+    (tree.header.near_node, tree.header.far_sides) = (1, 1);
+    tree.far = vec![tree.header.root.bounds(); far::SIDES];
+    let got = ordered(&tree, ChildOrder::LargerBox, tree.header.primitive_count);
+    assert_eq!((got.header.near_node, got.header.far_sides, got.far.len()), (0, 0, 0));
+    assert_as_on_the_host("with something far", &tree);
 }
 
 /// An order on the way is the order behind, but for the order in which areas are added up: the same work.

@@ -3,6 +3,7 @@
 use crate::common::{corpus, device};
 use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::far;
 use hedgerow::bvh::flux::{FluxGrid, GRID_BYTES};
 use hedgerow::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record, status};
 use hedgerow::bvh::reinsertion::{Cost, Probed, Reinsertion, ReinsertionOptions};
@@ -216,10 +217,13 @@ fn rays_teach_where_work_is_saved() {
 fn rounds_take_the_order_of_children_away() {
     let (_, positions, triangles) = corpus::random("random 500", 500, [0.0; 3], [1.0; 3]);
     let tree = lbvh::build(&positions, &triangles, Code::Mc30.full(), Collapse::SAH);
-    let tree = tree.in_child_order(ChildOrder::LargerBox, &Collapse::SAH);
+    let mut tree = tree.in_child_order(ChildOrder::LargerBox, &Collapse::SAH);
     assert_eq!(tree.header.child_order, 1);
+    // And what is told of something far, as subtrees may go there.
+    (tree.header.near_node, tree.header.far_sides) = (1, 1);
+    tree.far = vec![tree.header.root.bounds(); far::SIDES];
     let (got, _) = by_rays_on_device(&tree, &ReinsertionOptions::FAST, 0, None);
-    assert_eq!(got.header.child_order, 0);
+    assert_eq!((got.header.child_order, got.header.near_node, got.header.far_sides), (0, 0, 0));
     let expected = tree.reinserted_by(&ReinsertionOptions::FAST, 0, &CostOnHost::Area).expect("a tree");
     assert!(got.to_bytes() == expected.to_bytes());
 }

@@ -16,8 +16,7 @@ pub enum CodeBounds {
     /// of all boxes.
     Robust,
     /// The same, but what is far stands apart from all others, right below the root, where robust bounds put it into a corner of the core. For
-    /// trees in which rays begin at the rest ([`crate::bvh::far`]): in quantised nodes, whose cells are as coarse as a node is large, boxes
-    /// around both would be so, too; and in others tests of boxes are, that reach far.
+    /// trees in which rays begin at the rest ([`crate::bvh::far`]): a node around both would be met by nearly all of them.
     Apart,
 }
 
